@@ -257,7 +257,7 @@ class LagSearch:
         return _Sums(table[0], table[1], table[2], table[3:])
 
     def _at_every_lag(self) -> Iterator[_Lags]:
-        """Compare at every lag with the reference stretched by each skew, where enough bins are there for an overlap."""
+        """Compare at every lag with the reference stretched by each skew, where both have enough bins."""
         if self._too_short(self.own):
             return
         for skew in self.skews:

@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 EVERY: Final = 0.1
 """Time from one state to the next, s."""
 SENSOR: Final = 222
-"""Seed of the errors of an emulated device: always the same sensor, so that two calibrations of it agree. Its zero rate of
-1 to 2 deg/s is that of most such sensors; the 20 deg/s that the data sheet allows turn the attitude by 15 deg."""
+"""Seed of the errors of an emulated device: always the same sensor, so that two calibrations of it agree. Its zero rate
+of 1 to 2 deg/s is that of most such sensors; the 20 deg/s that the data sheet allows turn the attitude by 15 deg."""
 RESTS: Final = 100
 """Rests that are remembered: an hour of them on a screen of a minute."""
 
