@@ -220,6 +220,13 @@ def rotating(page: Page, folder: Path) -> None:
     page.wait_for_timeout(6000)
 
 
+def calibrated(page: Page, folder: Path) -> None:
+    """Look at the values at the end of a calibration."""
+    guided(page, folder)
+    page.get_by_test_id("values").wait_for(timeout=ROTATES_MS)
+    page.wait_for_timeout(1500)
+
+
 VIEWS: dict[str, Callable[[Page, Path], None]] = {
     view.__name__: view
     for view in (
@@ -242,6 +249,7 @@ VIEWS: dict[str, Callable[[Page, Path], None]] = {
         live,
         guided,
         rotating,
+        calibrated,
     )
 }
 

@@ -16,7 +16,7 @@ from imufit.log.columns import SENSOR_NAMES
 from imufit.loop import SensorModel
 from imufit.rests.poses import Pose
 from imufit.results.json_value import json_value
-from imufit.results.parameter import FAR, by_effect, parameter_frame, parameter_table
+from imufit.results.parameter import by_effect, parameter_frame, parameter_table, stands_out
 from imufit.results.part import Part
 from imufit.results.result import Result
 from imufit.results.table import Table
@@ -226,7 +226,7 @@ class SensorCalibration(Part):
     def shows_error(self) -> bool:
         """Whether a parameter lies so far from that of an ideal sensor that chance does not account for it."""
         return any(
-            abs(value) > FAR * self.standard_errors[effect][name] > 0.0
+            stands_out(value, self.standard_errors[effect][name])
             for effect, values in self.effects.items()
             for name, value in values.items()
         )

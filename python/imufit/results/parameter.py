@@ -153,6 +153,11 @@ def by_effect(parameters: Iterable[Parameter]) -> dict[str, dict[str, dict[str, 
     return effects
 
 
+def stands_out(value: float, standard_error: float) -> bool:
+    """Return whether a parameter lies so far from that of an ideal sensor that chance does not account for it."""
+    return abs(value) > FAR * standard_error > 0.0
+
+
 def in_lines(parameters: Sequence[Parameter], limit: int = 3) -> list[str]:
     """Write the parameters that stand out most from their errors, one each, and how many more there are."""
     if not parameters:

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from imufit import _imufit
 from imufit.errors import InputError
+from imufit.figures import quantity
 from imufit.lab.simulate import SCENARIOS
 from imufit.log.columns import SENSOR_NAMES
 from imufit.log.metadata import Frame
 from imufit.printable import printable
 from imufit.rests.poses import SIDES
 from imufit.results import Parameter
-from imufit.results.parameter import in_lines
-from imufit.results.phrasing import listed
+from imufit.results.parameter import stands_out
+from imufit.results.phrasing import capital, listed
 from imufit.studio.body import Body, angles_in_words, side_rotation
 from imufit.studio.heading import heading_of
 from imufit.studio.icons import light_or_dark, link_with_words
@@ -494,7 +495,7 @@ class _LivePage:
         self._result.clear()
         with self._result:
             for sentence in listening.calibrated:
-                ui.label(printable(sentence)).classes("text-sm").style("overflow-wrap: anywhere")
+                ui.label(printable(capital(sentence))).classes("text-sm").style("overflow-wrap: anywhere")
             _values(listening.estimated)
             model = listening.model
             if model is not None:
@@ -504,14 +505,32 @@ class _LivePage:
 
 
 def _values(parameters: Sequence[Parameter]) -> None:
-    """Lay out the parameters of each effect with their standard errors."""
+    """Lay out the parameters of each effect with their standard errors; effects that may be chance fold away."""
     by_effect: dict[str, list[Parameter]] = {}
     for item in parameters:
         by_effect.setdefault(item.effect, []).append(item)
-    with ui.element("div").classes("studio-live-values").props('data-testid="values"'):
-        for effect, items in by_effect.items():
-            heading_of(effect)
-            ui.label("; ".join(in_lines(items, len(items)))).classes("text-sm")
+    clear = {
+        effect
+        for effect, items in by_effect.items()
+        if any(stands_out(item.value, item.standard_error) for item in items)
+    }
+    with ui.element("div").classes("w-full").props('data-testid="values"'):
+        for effect in filter(clear.__contains__, by_effect):
+            _values_of(effect, by_effect[effect])
+        others = [effect for effect in by_effect if effect not in clear]
+        if others:
+            with ui.expansion(f"{quantity.counted(len(others), 'effect')} within the standard errors").props("dense"):
+                for effect in others:
+                    _values_of(effect, by_effect[effect])
+
+
+def _values_of(effect: str, parameters: Sequence[Parameter]) -> None:
+    """Lay out the parameters of one effect, one a line."""
+    heading_of(effect)
+    with ui.element("div").classes("studio-live-values"):
+        for item in parameters:
+            ui.label(item.name).classes("studio-muted")
+            ui.label(item.shown).classes("text-sm")
 
 
 def _attitude(angles: dict[str, Array]) -> tuple[str, Array | None]:
