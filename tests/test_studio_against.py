@@ -1,6 +1,8 @@
 """The list that a residual stands against, and the channel on which the figure opens."""
 
 import pytest
+from imufit.lab.simulate import simulate
+from imufit.results.comparison import OFFSET
 from imufit.results.sentences import leading
 from imufit.studio.against import SMALL, UNKNOWN, against, opens_on
 from imufit.studio.log_file import LogFile
@@ -48,6 +50,19 @@ def test_the_figure_opens_on_a_cause_where_no_covariate_shows_half_as_much(late)
     covariate = max((item for item in found.panels if item.channel == channel), key=lambda item: item.share).covariate
     assert opens_on(found, channel, None) == covariate
     assert opens_on(found, channel, {"domega/dt": 1.5 * best}) == covariate
+
+
+def test_an_offset_depends_on_nothing_and_opens_on_time(tmp_path):
+    """A cause that hardly varies must not pass for an offset: the size of the speed, for instance."""
+    log = simulate("handheld", {"acc.bias": {"x": 0.0, "y": 0.0, "z": -0.08}}, 3, duration=60.0, rate=50.0).to_log()
+    session = Session([log])
+    session.begin()
+    found, channel = session.compare(), "acc_z"
+    shares = session.weigh_causes()[channel]
+    assert max(shares.values()) < 0.1
+    assert opens_on(found, channel, shares) is None
+    offset = next(item for item in found.where if (item.channel, item.covariate) == (channel, OFFSET))
+    assert offset.share > 0.9
 
 
 def test_a_cause_without_a_share_yet_says_so(late):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache, partial
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,7 @@ def cause_names(analysis: Analysis, log: int, channel: str) -> tuple[str, ...]:
 
 
 def cause_shares(analysis: Analysis, step: Array, log: int, channels: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the part of each channel's excess that each cause explains, from the evidence alone: no row is read.
+    """Return the part of each channel's excess that each cause explains beside an offset; no row is read.
 
     Parameters
     ----------
@@ -59,22 +59,59 @@ def cause_shares(analysis: Analysis, step: Array, log: int, channels: Sequence[s
     """
     squares = analysis.problem.mean_squares(step, log)
     evidence = analysis.logs[log]
-    beside = cache(partial(analysis.problem.step_beside, analysis.fitted_slots))
+    fit_of = cache(partial(_fit_beside_offset, analysis, step, log))
     found: dict[str, dict[str, float]] = {}
     for channel in channels:
         excess = squares[channel] - evidence.floors[evidence.passes.channels.index(channel)] ** 2
         found[channel] = {}
         for cause, (slot, places) in _causes(analysis, log, channel).items():
-            left = analysis.problem.mean_squares(_moved(step, *beside(slot), places), log)[channel]
-            found[channel][cause] = min(max((squares[channel] - left) / excess, 0.0), 1.0)
+            fit = fit_of(slot)
+            both = _moved(step, [*fit.places, *(fit.own[k] for k in places)], fit.fitted)
+            without, left = (analysis.problem.mean_squares(at, log)[channel] for at in (fit.offset, both))
+            found[channel][cause] = min(max((without - left) / excess, 0.0), 1.0)
     return found
 
 
-def _moved(step: Array, own: Sequence[int], fitted: Array, places: Sequence[int]) -> Array:
-    """Return the step with a cause in it: some of the parameters of its slot, as they are fitted beside the model's."""
-    chosen = [own[k] for k in places]
+class _Fit(NamedTuple):
+    """A cause fitted beside the model and an offset of its sensor.
+
+    Around the mean, as covariates are judged: a residual that is constant depends on nothing, and a cause that hardly
+    varies would pass for it.
+    """
+
+    offset: Array
+    """Step of every parameter with the offset alone."""
+    places: list[int]
+    """Places of the offset's parameters."""
+    own: list[int]
+    """Places of the parameters of the cause's slot."""
+    fitted: Array
+    """Step of every parameter with both."""
+
+
+def _fit_beside_offset(analysis: Analysis, step: Array, log: int, slot: int) -> _Fit:
+    """Fit the slot of a cause beside the model, and beside an offset of its sensor if the model has none."""
+    problem, model = analysis.problem, list(analysis.fitted_slots)
+    sensors = analysis.logs[log].surveyed.probes[analysis.slots[slot]].sensors
+    offsets = [
+        analysis.slots.index(key)
+        for key, effect in analysis.candidates.items()
+        if effect.affine == "offset" and effect.sensors == sensors
+    ]
+    added = [each for each in offsets if each not in model]
+    offset, places = step, []
+    for each in added:
+        own, fitted = problem.step_beside(model, each)
+        offset = _moved(offset, own, fitted)
+        places += own
+    own, fitted = problem.step_beside([*model, *added], slot)
+    return _Fit(offset, places, own, fitted)
+
+
+def _moved(step: Array, places: Sequence[int], fitted: Array) -> Array:
+    """Return the step with some parameters as they are fitted besides."""
     moved = step.copy()
-    moved[chosen] += fitted[chosen]
+    moved[places] += fitted[places]
     return moved
 
 
@@ -105,7 +142,8 @@ def cause_panels(
     """
     slot, places = _causes(analysis, log, channel)[cause]
     evidence = analysis.logs[log]
-    moved = _moved(step, *analysis.problem.step_beside(analysis.fitted_slots, slot), places)
+    fit = _fit_beside_offset(analysis, step, log, slot)
+    moved = _moved(step, [fit.own[k] for k in places], fit.fitted)
     index = CHANNELS.index(channel)
     asked = [(analysis, step), (analysis, moved), *others]
     sources = [(each.logs[log].raw, each.own_step(log, at)) for each, at in asked]
