@@ -311,7 +311,7 @@ def main() -> None:
             print(view, flush=True)
         browser.close()
     if given.docs:
-        for view in IN_DOCS:
+        for view in (each for each in IN_DOCS if each in given.views):
             taken = Image.open(given.folder / f"{view}_1280_light.png").convert("RGB")
             small = taken.quantize(COLOURS, dither=Image.Dither.NONE)
             small.save(Path(__file__).parent / f"studio_{view}.png", optimize=True)
