@@ -13,6 +13,7 @@ from imufit.comparing.traces import STRETCHES
 from imufit.figures import quantity
 from imufit.report import page, pictures
 from imufit.results import Parameter
+from imufit.results.judged import Judged
 from loop_results import BIAS, G_SENSITIVITY, addition, comparison, diagnosis, ladder, noise, rows
 
 VOID = {"meta", "br", "link", "img", "hr", "input", "col"}
@@ -280,3 +281,13 @@ def test_hostile_names_of_columns_are_harmless_as_names_of_files():
     names = [picture.name for picture in pictures(replace(start, panels=panels))]
     assert len(names) == len(set(names))
     assert all(re.fullmatch(r"[A-Za-z0-9_]+", name) for name in names)
+
+
+def test_the_word_on_top_is_adequate_only_where_every_sensor_was_judged():
+    whole = diagnosis("adequate")
+    left = replace(whole, judged=(Judged("acc", False, "too few rests"),))
+    assert '<section class="verdict good">' in page(diagnosis=whole)
+    partly = page(diagnosis=left)
+    assert '<section class="verdict plain">' in partly
+    assert "<b>partly judged</b>" in partly
+    assert '<section class="verdict warn">' in page(diagnosis=diagnosis("missing"))

@@ -177,7 +177,8 @@ def _verdict(
     sentence = diagnosis.sentence or VERDICTS.get(diagnosis.verdict, "")
     if ladder is not None:
         sentence = ladder.sentence or sentence
-    return {"word": diagnosis.verdict, "kind": _KINDS.get(diagnosis.verdict, "plain"), "sentence": sentence}
+    word = diagnosis.headline.lower()
+    return {"word": word, "kind": _KINDS.get(word, "plain"), "sentence": sentence}
 
 
 def _judged(comparison: Comparison | None, diagnosis: Diagnosis | None) -> Table | None:
