@@ -693,6 +693,8 @@ def test_names_from_a_file_are_text(page, folder):
     marked(page, "covariate").click()
     # The share of the excess that the covariate explains stands behind its name.
     name = re.escape(HOSTILE[0]).replace("/", r"\/")
+    # The list draws what is in sight: typing brings the column there.
+    page.keyboard.type(f"{HOSTILE[0]} (")
     page.get_by_role("option", name=re.compile(rf"^{name} \((< )?[\d.]+ %\)$")).click()
     # The legend has the name of the effect that is looked at, too.
     title = "document.querySelector('[data-mark=panel] .xtitle')"
