@@ -6,7 +6,7 @@ Such a cause acts through several columns, so the residual stands against the pa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, partial
+from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -59,53 +59,48 @@ def cause_shares(analysis: Analysis, step: Array, log: int, channels: Sequence[s
     """
     squares = analysis.problem.mean_squares(step, log)
     evidence = analysis.logs[log]
-    fit_of = cache(partial(_fit_beside_offset, analysis, step, log))
+    beside = cache(analysis.problem.step_beside)
     found: dict[str, dict[str, float]] = {}
     for channel in channels:
         excess = squares[channel] - evidence.floors[evidence.passes.channels.index(channel)] ** 2
-        found[channel] = {}
-        for cause, (slot, places) in _causes(analysis, log, channel).items():
-            fit = fit_of(slot)
-            both = _moved(step, [*fit.places, *(fit.own[k] for k in places)], fit.fitted)
-            without, left = (analysis.problem.mean_squares(at, log)[channel] for at in (fit.offset, both))
+        causes, found[channel] = _causes(analysis, log, channel), {}
+        if not causes:
+            continue
+        offset = _offset(analysis, step, channel.partition("_")[0])
+        without = analysis.problem.mean_squares(offset.step, log)[channel]
+        for cause, (slot, places) in causes.items():
+            own, fitted = beside(offset.model, slot)
+            both = _moved(step, [*offset.places, *(own[k] for k in places)], fitted)
+            left = analysis.problem.mean_squares(both, log)[channel]
             found[channel][cause] = min(max((without - left) / excess, 0.0), 1.0)
     return found
 
 
-class _Fit(NamedTuple):
-    """A cause fitted beside the model and an offset of its sensor.
+class _Offset(NamedTuple):
+    """An offset of a sensor beside the model, unless the model has one.
 
-    Around the mean, as covariates are judged: a residual that is constant depends on nothing, and a cause that hardly
-    varies would pass for it.
+    Causes are fitted beside it, as covariates are judged about the mean: a residual that is constant depends on
+    nothing, and a cause that hardly varies would pass for it.
     """
 
-    offset: Array
-    """Step of every parameter with the offset alone."""
+    model: tuple[int, ...]
+    """Slots of the model, and that of the offset."""
     places: list[int]
     """Places of the offset's parameters."""
-    own: list[int]
-    """Places of the parameters of the cause's slot."""
-    fitted: Array
-    """Step of every parameter with both."""
+    step: Array
+    """Step of every parameter with the offset."""
 
 
-def _fit_beside_offset(analysis: Analysis, step: Array, log: int, slot: int) -> _Fit:
-    """Fit the slot of a cause beside the model, and beside an offset of its sensor if the model has none."""
-    problem, model = analysis.problem, list(analysis.fitted_slots)
-    sensors = analysis.logs[log].surveyed.probes[analysis.slots[slot]].sensors
-    offsets = [
-        analysis.slots.index(key)
-        for key, effect in analysis.candidates.items()
-        if effect.affine == "offset" and effect.sensors == sensors
-    ]
-    added = [each for each in offsets if each not in model]
-    offset, places = step, []
-    for each in added:
-        own, fitted = problem.step_beside(model, each)
-        offset = _moved(offset, own, fitted)
-        places += own
-    own, fitted = problem.step_beside([*model, *added], slot)
-    return _Fit(offset, places, own, fitted)
+def _offset(analysis: Analysis, step: Array, sensor: str) -> _Offset:
+    model, moved = tuple(analysis.fitted_slots), step
+    places: list[int] = []
+    for key, effect in analysis.candidates.items():
+        slot = analysis.slots.index(key)
+        if effect.affine == "offset" and list(effect.sensors) == [sensor] and slot not in model:
+            own, fitted = analysis.problem.step_beside(model, slot)
+            moved = _moved(moved, own, fitted)
+            model, places = (*model, slot), [*places, *own]
+    return _Offset(model, places, moved)
 
 
 def _moved(step: Array, places: Sequence[int], fitted: Array) -> Array:
@@ -142,8 +137,8 @@ def cause_panels(
     """
     slot, places = _causes(analysis, log, channel)[cause]
     evidence = analysis.logs[log]
-    fit = _fit_beside_offset(analysis, step, log, slot)
-    moved = _moved(step, [fit.own[k] for k in places], fit.fitted)
+    own, fitted = analysis.problem.step_beside(_offset(analysis, step, channel.partition("_")[0]).model, slot)
+    moved = _moved(step, [own[k] for k in places], fitted)
     index = CHANNELS.index(channel)
     asked = [(analysis, step), (analysis, moved), *others]
     sources = [(each.logs[log].raw, each.own_step(log, at)) for each, at in asked]

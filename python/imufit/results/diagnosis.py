@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from imufit.figures.place import Drawing, Place
 
 OFF_FLOOR: Final = 1.2
-"""Held-out error over the noise from which on a residual is no longer said to be at its noise floor."""
+"""Held-out error over the noise up to which a residual counts as at its noise floor."""
 VERDICTS = {
     "adequate": "Nothing that this log can show is missing.",
     "missing": "One effect is missing and stands out.",
@@ -298,9 +298,14 @@ class Diagnosis(Plotted, Result):
     @property
     def headline(self) -> str:
         """The verdict in capitals: ``ADEQUATE`` is for logs of which every sensor was judged and is at its noise."""
-        if self.verdict == "adequate" and not all(item.judged for item in self.judged):
-            return "PARTLY JUDGED"
-        return "ABOVE THE NOISE" if self.verdict == "adequate" and self.ratio > OFF_FLOOR else self.verdict.upper()
+        if self.verdict != "adequate" or self.whole:
+            return self.verdict.upper()
+        return "ABOVE THE NOISE" if all(item.judged for item in self.judged) else "PARTLY JUDGED"
+
+    @property
+    def whole(self) -> bool:
+        """Whether every sensor was judged, and the residual is at its noise floor."""
+        return all(item.judged for item in self.judged) and not self.ratio > OFF_FLOOR
 
     @property
     def best_candidate(self) -> Candidate | None:

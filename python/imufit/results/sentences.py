@@ -94,7 +94,7 @@ def _adequate(found: Diagnosis, untold: int) -> str:
     rests = "rests" in found.evidence
     if found.ratio > OFF_FLOOR:
         return (
-            f"{'Without a reference attitude no' if rests else 'No'} effect is missing for certain, but the residual "
+            f"No effect is missing for certain{' without a reference attitude' if rests else ''}, but the residual "
             f"stands at {found.ratio:.2f} times the noise: the noise is stronger or more coloured than stated, or the "
             "log does not contain the cause of the residual."
         )

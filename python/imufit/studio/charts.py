@@ -118,7 +118,7 @@ def residual_panel(
     after: Panel | None = None,
     other: Panel | None = None,
     *,
-    effect: str = "this effect",
+    effect: str = "",
     explained: bool = False,
 ) -> Figure:
     """Draw the residual of one channel against one covariate.

@@ -500,7 +500,7 @@ def _icon_of(diagnosis: Diagnosis) -> str:
     if diagnosis.contradicted:
         return ICONS["unknown"]
     # The tick is for a whole model: every sensor was judged, and no residual stands above its noise.
-    return ICONS[diagnosis.verdict] if diagnosis.headline == diagnosis.verdict.upper() else PART_JUDGED
+    return ICONS[diagnosis.verdict] if diagnosis.whole or diagnosis.verdict != "adequate" else PART_JUDGED
 
 
 def _named(desk: Desk) -> str:
